@@ -3,8 +3,10 @@
 // METHOD   a model without the block of the only hit knows nothing of a mode: that it stands elsewhere means nothing. The deviation
 //          is then that of a least-squares fit (Cramer-Rao bound). Its regressors are the motion q of each mode, whose factors are
 //          the shapes, the forces, whose factor is D, and d, the derivative of q by the pole. The noise is what the model leaves,
-//          correlated with d beside the mode's frequency; at the frequency itself the fit has left nothing. The median distance
-//          of the runs from the values is added, as a root of squares
+//          correlated with d beside the mode's frequency; at the frequency itself the fit has left nothing. There the noise is
+//          larger where it shakes the structure as traffic does: a + b / (1 + x^2) at x half-widths from the frequency, a and b
+//          from what is left near to it and far from it. The median distance of the runs from the values is added, as a root of
+//          squares
 #include "fit_deviation.hpp"
 
 #include "modal_answer.hpp"
@@ -26,9 +28,12 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr std::size_t event_blocks = 20;                   // as a jackknife leaves out
-constexpr std::array half_widths_away{2.0, 3.0, 4.0, 5.0}; // half-power half-widths from the frequency, on both sides
-constexpr double silent = 1e-12;                           // of the largest power: what comes later adds nothing
+constexpr std::size_t event_blocks = 20; // as a jackknife leaves out
+// half-power half-widths from the frequency, on both sides
+constexpr std::array near_lines{1.5, 2.5, 3.5}, far_lines{5.0, 7.0, 9.0};
+constexpr double shaken_share = 0.75; // of b in the pole's noise: (1 + x^2)^-3 over (1 + x^2)^-2, integrals over x
+constexpr double near_over_far = 0.6; // deviation of near over far of one output, where b is 0: 6 lines each
+constexpr double silent = 1e-12;      // of the largest power: what comes later adds nothing
 constexpr Index gram_rows = 256;
 
 /// The largest share of one block.
@@ -49,14 +54,36 @@ bool has_event(const record_set& set) {
                        [](const auto& of_block) { return largest_share(of_block) > most_of_one_block; });
 }
 
+/// Mean of 1 / (1 + x^2).
+double shaken_at(const std::array<double, 3>& half_widths) {
+    double sum = 0;
+    for (const double x : half_widths) sum += 1 / (1 + x * x);
+    return sum / half_widths.size();
+}
+
+/// What is left beside a mode, of each output, summed over so many records.
+struct left_beside {
+    VectorXd near_it, far_from_it;
+    double records = 0;
+
+    /// Power at the mode. How much of it the structure amplifies is the same for all outputs.
+    VectorXd at_the_mode() const {
+        const double by_near = shaken_at(near_lines), by_far = shaken_at(far_lines);
+        const double ratio = (near_it.array() / far_from_it.array().max(1e-300)).mean(),
+                     by_chance = near_over_far / std::sqrt(records * static_cast<double>(near_it.size()));
+        const double b = std::max(0.0, ratio - 1 - by_chance) / (by_near - by_far); // over what is far from it
+        return (near_it + far_from_it) / 2 + (shaken_share - (by_near + by_far) / 2) * b * far_from_it;
+    }
+};
+
 /// What a fit of shapes, D and poles knows, summed over the records.
 struct fit_sums {
     const record_work& work;
     std::vector<const listed_mode*> modes;
     MatrixXd gram;                             ///< of Re q, Im q of each mode, the forces, Re d, Im d of each mode
     std::vector<std::vector<double>> of_block; ///< energy of d, of each mode
-    std::vector<VectorXd> heard,
-        noise; ///< of each mode and output: energy of d where it was measured, power of what is left
+    std::vector<VectorXd> heard;               ///< of each mode and output: energy of d where it was measured
+    std::vector<left_beside> left;             ///< of each mode
 
     Index linear() const { return static_cast<Index>(2 * modes.size() + work.set.n_u); }
 
@@ -95,7 +122,7 @@ struct fit_sums {
         }
     }
 
-    /// Correlation of what is left with d, turned beside the mode's frequency.
+    /// Correlations of what is left with d, turned beside the mode's frequency.
     void add_noise(const answered_record& record, const std::vector<complex>& d, std::size_t k) {
         const std::size_t n_y = work.set.n_y;
         const double half = 2 * M_PI * modes[k]->frequency_hz * modes[k]->damping_ratio * work.model.dt;
@@ -106,7 +133,15 @@ struct fit_sums {
         for (std::size_t t = 0; t < end; ++t)
             for (std::size_t o = 0; o < n_y; ++o)
                 if (!std::isnan(record.left[t * n_y + o])) heard[k][static_cast<Index>(o)] += std::norm(d[t]);
-        for (const double away : half_widths_away)
+        add_left(record, d, end, half, near_lines, left[k].near_it);
+        add_left(record, d, end, half, far_lines, left[k].far_from_it);
+        ++left[k].records;
+    }
+
+    void add_left(const answered_record& record, const std::vector<complex>& d, std::size_t end, double half,
+                  const std::array<double, 3>& half_widths, VectorXd& power) const {
+        const std::size_t n_y = work.set.n_y;
+        for (const double away : half_widths)
             for (const double side : {-away, away}) {
                 const complex step = std::polar(1.0, side * half);
                 complex turn = 1;
@@ -114,10 +149,10 @@ struct fit_sums {
                 for (std::size_t t = 0; t < end; ++t, turn *= step) {
                     const complex with = std::conj(d[t]) * turn;
                     for (std::size_t o = 0; o < n_y; ++o)
-                        if (const double left = record.left[t * n_y + o]; !std::isnan(left)) sum[o] += with * left;
+                        if (const double y = record.left[t * n_y + o]; !std::isnan(y)) sum[o] += with * y;
                 }
                 for (std::size_t o = 0; o < n_y; ++o)
-                    noise[k][static_cast<Index>(o)] += std::norm(sum[o]) / (2.0 * half_widths_away.size());
+                    power[static_cast<Index>(o)] += std::norm(sum[o]) / (2.0 * half_widths.size());
             }
     }
 };
@@ -210,7 +245,9 @@ void deviations_by_fit(const std::vector<listed_mode>& listed, record_work& work
     const Index size = sums.linear() + static_cast<Index>(2 * place.size());
     sums.gram = MatrixXd::Zero(size, size);
     sums.of_block.assign(place.size(), std::vector<double>(event_blocks));
-    sums.heard = sums.noise = std::vector<VectorXd>(place.size(), VectorXd::Zero(static_cast<Index>(n_y)));
+    const VectorXd none = VectorXd::Zero(static_cast<Index>(n_y));
+    sums.heard.assign(place.size(), none);
+    sums.left.assign(place.size(), {none, none});
     for (std::size_t r = 0; r < work.set.records.size(); ++r) sums.add(r);
     const fit_information information(sums);
     for (std::size_t k = 0; k < place.size(); ++k) {
@@ -218,10 +255,11 @@ void deviations_by_fit(const std::vector<listed_mode>& listed, record_work& work
         const std::vector<double>& of_block = sums.of_block[k];
         const bool of_event = event && largest_share(of_block) >= most_of_one_block;
         if (!std::isnan(sigma.frequency_hz[i]) && !of_event) continue;
-        if (!(sums.heard[k].minCoeff() > 0) || !(sums.noise[k].minCoeff() > 0)) continue;
+        const VectorXd left = sums.left[k].at_the_mode();
+        if (!(sums.heard[k].minCoeff() > 0) || !(left.minCoeff() > 0)) continue;
         // as if all samples had been measured: fewer tell less
         const double energy = std::accumulate(of_block.begin(), of_block.end(), 0.0);
-        const VectorXd noise = energy * sums.noise[k].array() / sums.heard[k].array().square();
+        const VectorXd noise = energy * left.array() / sums.heard[k].array().square();
         const auto [f, zeta] = of_values(listed[i], of_pole(sums, information.of_poles, noise, k));
         // a run through the model ends where a force is missing, which may be too early to tell anything
         if (!(f > 0) || !(zeta > 0) || !(f < 0.5 / work.model.dt) || !(zeta < 1)) continue;

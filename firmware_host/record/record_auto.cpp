@@ -12,6 +12,7 @@
 #include "consensus/quantity.hpp"
 #include "error.hpp"
 #include "fit_deviation.hpp"
+#include "late_force.hpp"
 #include "looks.hpp"
 #include "modal_gain.hpp"
 #include "modal_model.hpp"
@@ -447,7 +448,6 @@ record_result identify_auto(record_set records, const record_options& given, con
     work.before = before && before->samples() > 0 ? before : split.get();
     const missing_count asked = count_missing(work.set);
     check_measured(asked, work.set, given);
-    const long long asked_gaps = asked.gaps;
     screened_outputs screened = screen_outputs(work.set, given.outputs);
     const bool all = std::all_of(screened.kept.begin(), screened.kept.end(), [](bool kept) { return kept; });
     if (!all) work.set = without_outputs(work.set, screened.kept);
@@ -462,12 +462,13 @@ record_result identify_auto(record_set records, const record_options& given, con
         check_different_inputs(moments_of(work.set), options); // else they need not have been alike before
     const missing_count missing = count_missing(work.set);
     work.context = describe_records(work.set, options, missing);
-    if (asked_gaps == 0) work.context.warnings.clear(); // the gaps are those screened
+    if (asked.gaps == 0) work.context.warnings.clear(); // the gaps are those screened
     work.context.warnings.insert(work.context.warnings.end(), repeated.begin(), repeated.end());
     if (work.before)
-        work.before->add_counts(asked_gaps > 0 ? missing : missing_count(), work.set.count(), work.context);
+        work.before->add_counts(asked.gaps > 0 ? missing : missing_count(), work.set.count(), work.context);
     work.context.warnings.insert(work.context.warnings.end(), screened.said.begin(), screened.said.end());
     remark_changed_output(work.set, work.context);
+    if (!work.before) bring_force_forward(work.set, options.fs_hz, work.context.warnings);
     work.at_rest = begin_at_rest(work.set, options);
     if (work.at_rest) work.context.start = "rest";
     if (options.detrend == "linear") detrend_linear(work.set, options);

@@ -41,14 +41,6 @@ double middle_of(const record_set& set, const record_data& record, std::size_t c
     return values.empty() ? 0 : upper_median(values);
 }
 
-/// A channel less what it rests at.
-std::vector<double> from_rest(const record_set& set, const record_data& record, std::size_t channel) {
-    const double rest = middle_of(set, record, channel);
-    std::vector<double> out(record.count);
-    for (std::size_t i = 0; i < record.count; ++i) out[i] = set.rows(record)[i * set.channels() + channel] - rest;
-    return out;
-}
-
 /// Samples of a force that differ from rest by more than `least`, in stretches.
 std::vector<std::pair<std::size_t, std::size_t>> stretches_beyond(const std::vector<double>& force, double least) {
     std::vector<std::pair<std::size_t, std::size_t>> out;
@@ -148,6 +140,15 @@ force_level level_of(const double* force, std::size_t stride, std::size_t count)
     out.rests = beyond * resting_share <= count;
     return out;
 }
+
+std::vector<double> from_rest(const record_set& set, const record_data& record, std::size_t channel) {
+    const double rest = middle_of(set, record, channel);
+    std::vector<double> out(record.count);
+    for (std::size_t i = 0; i < record.count; ++i) out[i] = set.rows(record)[i * set.channels() + channel] - rest;
+    return out;
+}
+
+bool acts_in_hits(const std::vector<double>& force) { return !hits_of(force).acts.empty(); }
 
 bool begins_at_rest(const record_set& set, const record_data& record) {
     const std::size_t hit = onset(set, record);

@@ -12,6 +12,12 @@ struct force_level {
 };
 force_level level_of(const double* force, std::size_t stride, std::size_t count);
 
+/// A channel of a record less what it rests at.
+std::vector<double> from_rest(const record_set& set, const record_data& record, std::size_t channel);
+
+/// Does a force act in hits alone, each of one sign? @param force  less what it rests at, NaN: missing
+bool acts_in_hits(const std::vector<double>& force);
+
 /// Is a record silent before its force sets in?
 bool begins_at_rest(const record_set& set, const record_data& record);
 

@@ -105,9 +105,11 @@ constexpr double falling = 0.1; ///< steps down less steps up of an amplitude, o
 constexpr double stronger = 10; ///< amplitude of the vibration over that of its multiple
 constexpr double product_periods = 6;  ///< in a block, of the slowest factor
 constexpr double machine_periods = 32; ///< in a block at most, to see a tone and its multiples
-constexpr double force_line = 10;      ///< power of a line of the force over that beside it
-constexpr double force_ends = 100;     ///< power of a force over that beyond the edge of its band
-constexpr double resonance_peak = 2;   ///< power of the responses, over that of the force, at a mode over beside it
+constexpr double answered_before =
+    1.5;                           ///< power left of an output, over that with the next sample of the force: it is late
+constexpr double force_line = 10;  ///< power of a line of the force over that beside it
+constexpr double force_ends = 100; ///< power of a force over that beyond the edge of its band
+constexpr double resonance_peak = 2; ///< power of the responses, over that of the force, at a mode over beside it
 
 // Distortion: products of stronger vibrations.
 constexpr std::size_t product_blocks = 16;    ///< to speak of a coherence

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import okid
+import pytest
 import scipy.signal
 from numpy.typing import NDArray
 
@@ -82,3 +83,25 @@ def test_a_channel_that_comes_back_slowly_moves_no_mode() -> None:
     assert share < 1e-6 and z < 2  # from the agreement alone 1.1e-5 and 2.7
     u, y = struck(8, 0.0)
     assert "force_window" not in codes(okid.identify(u, y, fs=FS))
+
+
+def recorded(seed: int, late: float) -> tuple[Real, Real]:
+    """The force comes so many samples late."""
+    u, y = struck(seed, 0.02)
+    turn = np.exp(-2j * np.pi * np.fft.rfftfreq(len(u), 1 / FS) * late / FS)
+    return np.fft.irfft(np.fft.rfft(u[:, 0]) * turn, len(u))[:, None], y
+
+
+@pytest.mark.parametrize("late", [3, 25, 5.3])
+def test_a_late_force_is_taken_forward(late: float) -> None:
+    """What it says is what it says without the delay, up to a part of a sample."""
+    sound, found = (okid.identify(*recorded(3, samples), fs=FS) for samples in (0, late))
+    assert "late_force" not in codes(sound)
+    said = next(one.text for one in found.warnings if one.code == "late_force")
+    assert f" {late:.0f} samples ({late:.0f} ms) late" in said
+    assert len(found.confident_modes) == len(TRUE)
+    for mode, other in zip(found.confident_modes, sound.confident_modes, strict=True):
+        assert mode.frequency_hz == pytest.approx(other.frequency_hz, rel=1e-5)
+        assert mode.damping_ratio == pytest.approx(other.damping_ratio, rel=1e-2)
+    if late == int(late):
+        assert found.fit.simulation_percent == pytest.approx(sound.fit.simulation_percent, abs=0.01)
