@@ -88,6 +88,7 @@ class future_fit {
     static constexpr Index rows_per_column = 4;
 
     void take(const Eigen::Ref<const MatrixXd>& rows) {
+        if (rows.cols() == 0) return;
         gram_.selfadjointView<Eigen::Lower>().rankUpdate(rows);
         rows_ += rows.cols();
     }

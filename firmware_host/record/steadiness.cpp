@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
 // PURPOSE  modes whose frequency depends on the level of vibration or changes while it is recorded
 // METHOD   the frequency of a mode in short blocks, as a straight line over the mode's power and over time. With a force: the
-//          correction of the pole that explains a block's residual best (one Gauss-Newton step, its own initial state free).
-//          Without: the turning of the mode's analytic signal; of a linear structure under Gaussian forces its mean does not
-//          depend on the envelope (Rice 1945). The deviation of the slopes comes from the scatter about the line; a slope
-//          must remain without the blocks that weigh most, those of one gust or one hit
+//          correction of the pole that explains a block's residual best (one Gauss-Newton step, its own initial state free), of a
+//          weight by what it leaves there: errors of the model are loud where the structure is, as after a hit. Without: the
+//          turning of the mode's analytic signal; of a linear structure under Gaussian forces its mean does not depend on the
+//          envelope (Rice 1945). The deviation of the slopes comes from the scatter about the line, that of all blocks or that
+//          where the evidence is (White 1980), whichever is larger; a slope must remain without the blocks that weigh most,
+//          those of one gust or one hit
 #include "steadiness.hpp"
 
 #include "files/order_statistics.hpp"
@@ -33,6 +35,8 @@ constexpr double worth_saying = 0.02;   // change over the half-power bandwidth
 constexpr double widest = 0.1;          // damping above: nothing repeats over a block
 constexpr double alone = 4;             // bandwidths to the next mode or tone, without a force
 constexpr double outstanding = 2;       // a mode over what the model leaves: below, that is mostly something else
+constexpr double least_left = 1e-9;     // of what is left in a block, behind its own correction: rounding
+constexpr double a_group = 1.0 / 40;    // of the weight: neighbouring blocks of that much scatter together
 constexpr double throughout = 0.5;      // of the time, in which the middle 90 % of the evidence on a drift lie
 
 /// The frequency of a mode in one block, relative to that of the model.
@@ -55,6 +59,26 @@ double time_covered(const std::vector<block_frequency>& over) {
         sum += b.weight;
     }
     return (last - first) / (over.back().time - over.front().time);
+}
+
+/// Covariance of the slopes where the scatter is larger in some blocks than in others, neighbours taken together.
+Matrix3d where_evidence_is(const std::vector<block_frequency>& over, double block_frequency::* level,
+                           const Vector3d& mean, const Vector3d& slope, const Matrix3d& inverse) {
+    double total = 0, squares = 0, together = 0;
+    for (const block_frequency& b : over) total += b.weight, squares += b.weight * b.weight;
+    Matrix3d sum = Matrix3d::Zero();
+    Vector3d group = Vector3d::Zero();
+    for (const block_frequency& b : over) {
+        const Vector3d x = Vector3d(1, b.*level, b.time) - mean;
+        group += b.weight * (b.change - slope.dot(x)) * x;
+        together += b.weight;
+        if (together <= a_group * total && &b != &over.back()) continue;
+        sum += group * group.transpose();
+        group.setZero();
+        together = 0;
+    }
+    const double alike = total * total / squares; // blocks of equal weight
+    return inverse * sum * inverse * (alike / (alike - 3));
 }
 
 /// Weighted line over a power and time; changes from the quietest to the loudest tenth, and from begin to end.
@@ -89,8 +113,9 @@ slopes slopes_of(const std::vector<block_frequency>& over, double block_frequenc
     if (!inverse.allFinite() || !(scatter > 0)) return out;
     out.level = slope[1] * (quantile(powers, 0.9) - quantile(powers, 0.1));
     out.drift = slope[2] * (quantile(times, 1) - quantile(times, 0));
-    out.level_ratio = std::abs(slope[1]) / std::sqrt(scatter * inverse(1, 1));
-    out.drift_ratio = std::abs(slope[2]) / std::sqrt(scatter * inverse(2, 2));
+    const Matrix3d uneven = where_evidence_is(over, level, mean, slope, inverse);
+    out.level_ratio = std::abs(slope[1]) / std::sqrt(std::max(scatter * inverse(1, 1), uneven(1, 1)));
+    out.drift_ratio = std::abs(slope[2]) / std::sqrt(std::max(scatter * inverse(2, 2), uneven(2, 2)));
     return out;
 }
 
@@ -101,6 +126,7 @@ std::vector<block_frequency> without_heaviest(std::vector<block_frequency> over)
     for (const block_frequency& b : over) total += b.weight, squares += b.weight * b.weight;
     const double heavy = decisive * total * total / squares;
     over.resize(over.size() - std::min(over.size(), static_cast<std::size_t>(std::ceil(heavy))));
+    std::sort(over.begin(), over.end(), [](const auto& a, const auto& b) { return a.time < b.time; });
     return over;
 }
 
@@ -139,6 +165,7 @@ std::vector<double> motion_of(const steady_search& s, const answered_record& rec
 struct pole_equations {
     Eigen::Matrix4d N = Eigen::Matrix4d::Zero(); ///< of Re a, Im a, Re b, Im b
     Eigen::Vector4d h = Eigen::Vector4d::Zero();
+    double power = 0, values = 0; ///< of left: sum of squares, and of how many
 
     /// One sample. squares: weighted sum of |c|^2, turned: of c^2, seen: of c left.
     void add(complex p, complex s, double squares, complex turned, complex seen) {
@@ -175,6 +202,8 @@ block_frequency corrected(const steady_search& s, const answered_record& record,
             squares += std::norm(c);
             turned += c * c;
             seen += c * (left / s.spread[o]);
+            sums.power += left * left / s.spread[o] / s.spread[o];
+            ++sums.values;
         }
         sums.add(p, start, squares, turned, seen);
         const complex q = record.states[k][t];
@@ -189,8 +218,10 @@ block_frequency corrected(const steady_search& s, const answered_record& record,
     const Eigen::Matrix4d inverse = scaled.inverse();
     const Eigen::Vector4d x = inverse * sums.h.cwiseQuotient(size);
     const double w = 2 * M_PI * s.modes[k]->frequency_hz;
+    const double after =
+        std::max(least_left * sums.power, sums.power - x.dot(sums.h.cwiseQuotient(size))) / sums.values;
     return {x[0] / size[0] / w, power, motion / static_cast<double>(length), time,
-            size[0] * size[0] / inverse(0, 0) * w * w};
+            after > 0 ? size[0] * size[0] / inverse(0, 0) * w * w / after : 0};
 }
 
 std::size_t block_length(const listed_mode& mode, double fs_hz) {

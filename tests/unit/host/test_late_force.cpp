@@ -64,6 +64,18 @@ void others_are_not() {
     TEST_ASSERT_EQUAL_UINT64(0, found(17, 10)); // nothing tells
 }
 
+/// As many samples as a multiple of what is taken at a time.
+void any_number_of_samples_will_do() {
+    const series all = hammer(3), outputs = answer_to(all, 4, 1e-3);
+    for (std::size_t samples = 1000; samples < 1300; ++samples) {
+        const auto end = static_cast<std::ptrdiff_t>(samples);
+        const series late = later(all, 12);
+        TEST_ASSERT_EQUAL_UINT64(
+            12, samples_late(record_of(
+                    {series(late.begin(), late.begin() + end), series(outputs.begin(), outputs.begin() + end)}, 1)));
+    }
+}
+
 /// One of three outputs that is early is a matter of its own.
 void half_of_the_outputs_say_so() {
     const series force = hammer(3);
@@ -118,6 +130,7 @@ int main() {
     UNITY_BEGIN();
     RUN_TEST(a_late_force_is_late_by_so_many_samples);
     RUN_TEST(others_are_not);
+    RUN_TEST(any_number_of_samples_will_do);
     RUN_TEST(half_of_the_outputs_say_so);
     RUN_TEST(forces_that_are_no_hits_are_not_judged);
     RUN_TEST(the_force_is_taken_forward);
