@@ -204,7 +204,8 @@ record_result identify_files_of_samples(identify_arguments given) {
         given.references.empty() ? std::vector<std::string>() : split_names("--references", given.references);
     if (given.set_ups && given.records.size() < 2) usage("--setups: found one file, expected one for each set-up");
     if (given.set_ups && !(given.places.empty() && given.wanted.hit_dofs.empty()))
-        usage("--setups says that sensors were moved, --places and --hit-dofs that the hammer was: leave one out");
+        usage("--setups says that sensors were moved, --places and --hit-dofs that the hammer was: leave one out. If "
+              "both were, identify each place of the sensors with --places --json, and join the results: okid merge");
     given.wanted.set_ups = given.set_ups;
     if (!given.places.empty()) {
         if (!given.wanted.hit_dofs.empty())

@@ -29,8 +29,7 @@ TRUE = {
     | {f"frame3_flex_{name}" for name in ("sine10", "sine15", "sine20", "decay")},
     "unexplained": {"plane_lab1_1"},  # 17.5 Hz, a side band of the first mode: listed as doubtful
 }  # fmt: skip
-# Of a tower, and 0.002 % at 105.2 Hz of an aircraft.
-UNKNOWN = {("level_dependent", name) for name in ("tower_wn2", "plane_lab1_1")}
+UNKNOWN = {("level_dependent", "tower_wn2")}
 MUST = {("level_dependent", "silverbox_multisine"), ("level_dependent", "silverbox_arrow"), ("screened", "tower_wn1")}
 
 
