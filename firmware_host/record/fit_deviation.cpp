@@ -9,6 +9,7 @@
 //          squares
 #include "fit_deviation.hpp"
 
+#include "gram_sum.hpp"
 #include "modal_answer.hpp"
 #include "record_uncertainty.hpp"
 #include "result/judgement.hpp"
@@ -34,7 +35,6 @@ constexpr std::array near_lines{1.5, 2.5, 3.5}, far_lines{5.0, 7.0, 9.0};
 constexpr double shaken_share = 0.75; // of b in the pole's noise: (1 + x^2)^-3 over (1 + x^2)^-2, integrals over x
 constexpr double near_over_far = 0.6; // deviation of near over far of one output, where b is 0: 6 lines each
 constexpr double silent = 1e-12;      // of the largest power: what comes later adds nothing
-constexpr Index gram_rows = 256;
 
 /// The largest share of one block.
 double largest_share(const std::vector<double>& of_block) {
@@ -80,7 +80,7 @@ struct left_beside {
 struct fit_sums {
     const record_work& work;
     std::vector<const listed_mode*> modes;
-    MatrixXd gram;                             ///< of Re q, Im q of each mode, the forces, Re d, Im d of each mode
+    gram_sum gram;                             ///< of Re q, Im q of each mode, the forces, Re d, Im d of each mode
     std::vector<std::vector<double>> of_block; ///< energy of d, of each mode
     std::vector<VectorXd> heard;               ///< of each mode and output: energy of d where it was measured
     std::vector<left_beside> left;             ///< of each mode
@@ -103,23 +103,20 @@ struct fit_sums {
             }
         }
         for (std::size_t k = 0; k < modes.size(); ++k) add_noise(record, d[k], k);
-        MatrixXd rows(gram.rows(), gram_rows);
-        for (std::size_t first = 0; first < record.count; first += gram_rows) {
-            const Index count = std::min<Index>(gram_rows, static_cast<Index>(record.count - first));
-            for (Index i = 0; i < count; ++i) {
-                const std::size_t t = first + static_cast<std::size_t>(i);
-                for (Index k = 0; k < n_m; ++k) {
-                    const auto at = static_cast<std::size_t>(k);
-                    rows(2 * k, i) = record.states[at][t].real();
-                    rows(2 * k + 1, i) = record.states[at][t].imag();
-                    rows(linear() + 2 * k, i) = d[at][t].real();
-                    rows(linear() + 2 * k + 1, i) = d[at][t].imag();
-                }
-                const double* u = set.rows(set.records[r]) + t * set.channels();
-                for (Index j = 0; j < n_u; ++j) rows(2 * n_m + j, i) = u[j];
+        for (std::size_t t = 0; t < record.count; ++t) {
+            auto x = gram.next();
+            for (Index k = 0; k < n_m; ++k) {
+                const auto at = static_cast<std::size_t>(k);
+                x[2 * k] = record.states[at][t].real();
+                x[2 * k + 1] = record.states[at][t].imag();
+                x[linear() + 2 * k] = d[at][t].real();
+                x[linear() + 2 * k + 1] = d[at][t].imag();
             }
-            gram.selfadjointView<Eigen::Lower>().rankUpdate(rows.leftCols(count));
+            const double* u = set.rows(set.records[r]) + t * set.channels();
+            for (Index j = 0; j < n_u; ++j) x[2 * n_m + j] = u[j];
+            gram.keep();
         }
+        gram.fold();
     }
 
     /// Correlations of what is left with d, turned beside the mode's frequency.
@@ -157,24 +154,13 @@ struct fit_sums {
     }
 };
 
-/// A symmetric matrix with a unit diagonal: what it was divided by is the square of `size`.
-struct scaled_matrix {
-    VectorXd size;
-    MatrixXd values;
-
-    explicit scaled_matrix(const MatrixXd& given) : size(given.diagonal().cwiseMax(1e-300).cwiseSqrt()) {
-        const VectorXd unit = size.cwiseInverse();
-        values = unit.asDiagonal() * given * unit.asDiagonal();
-    }
-};
-
 /// The Gram matrix of d less what shapes and D explain of it, and the inverse of theirs.
 struct fit_information {
     MatrixXd of_poles;
     VectorXd of_shapes; ///< its diagonal
 
     explicit fit_information(const fit_sums& sums) {
-        const scaled_matrix gram(sums.gram.selfadjointView<Eigen::Lower>());
+        const scaled_matrix gram(sums.gram.values());
         const Index linear = sums.linear(), poles = gram.size.size() - linear;
         const auto explained = gram.values.topLeftCorner(linear, linear).ldlt();
         const MatrixXd across = gram.values.topRightCorner(linear, poles);
@@ -230,7 +216,7 @@ void deviations_by_fit(const std::vector<listed_mode>& listed, record_work& work
     result_context& context = work.context;
     if (work.set.n_u == 0 || !context.sigma || !context.x0 || work.before) return;
     deviations& sigma = *context.sigma;
-    fit_sums sums{work, {}, {}, {}, {}, {}};
+    fit_sums sums{work, {}, gram_sum(0), {}, {}, {}};
     std::vector<std::size_t> place; // in the list, of a mode of the model
     bool missing = false;
     for (std::size_t i = 0; i < listed.size(); ++i) {
@@ -243,7 +229,7 @@ void deviations_by_fit(const std::vector<listed_mode>& listed, record_work& work
     if (place.empty() || (!missing && !event)) return;
     const std::size_t n_y = work.set.n_y;
     const Index size = sums.linear() + static_cast<Index>(2 * place.size());
-    sums.gram = MatrixXd::Zero(size, size);
+    sums.gram = gram_sum(size);
     sums.of_block.assign(place.size(), std::vector<double>(event_blocks));
     const VectorXd none = VectorXd::Zero(static_cast<Index>(n_y));
     sums.heard.assign(place.size(), none);

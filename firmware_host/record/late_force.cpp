@@ -6,6 +6,7 @@
 //          the precursor of a linear-phase filter
 #include "late_force.hpp"
 
+#include "gram_sum.hpp"
 #include "record_rest.hpp"
 #include "result/judgement.hpp"
 
@@ -20,13 +21,11 @@ namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 constexpr std::size_t lags_before = 40, most_late = 64, allowed_after = 2;
 constexpr std::size_t most_rows = 20000, fewest_after_a_hit = 300;
 constexpr std::size_t outputs_asked = 3;
-constexpr Index rows_at_a_time = 256;
-constexpr double ridge_of_unit = 1e-10; // of a unit diagonal
+constexpr double ridge_of_unit = 1e-10;
 
 /// Samples about the hits, in order, `most` at most.
 std::vector<std::size_t> about_hits(const std::vector<double>& force, std::size_t most) {
@@ -47,54 +46,42 @@ std::vector<std::size_t> about_hits(const std::vector<double>& force, std::size_
     return out;
 }
 
-/// Gram matrix of an output's regressors and, last, the output.
+/// Least squares of an output by itself before and by the force before and after.
 class future_fit {
   public:
     void add(const std::vector<double>& force, const std::vector<double>& output,
              const std::vector<std::size_t>& samples) {
-        MatrixXd rows(columns, rows_at_a_time);
-        Index count = 0;
         for (const std::size_t n : samples) {
+            auto x = sum_.next();
             Index at = 0;
-            for (std::size_t back = 1; back <= lags_before; ++back) rows(at++, count) = output[n - back];
-            for (std::size_t i = n - lags_before; i <= n + most_late; ++i) rows(at++, count) = force[i];
-            rows(at, count) = output[n];
-            if (!rows.col(count).allFinite()) continue;
-            if (++count < rows_at_a_time) continue;
-            take(rows.leftCols(count));
-            count = 0;
+            for (std::size_t back = 1; back <= lags_before; ++back) x[at++] = output[n - back];
+            for (std::size_t i = n - lags_before; i <= n + most_late; ++i) x[at++] = force[i];
+            x[at] = output[n];
+            if (x.allFinite()) sum_.keep();
         }
-        take(rows.leftCols(count));
+        sum_.fold();
     }
 
     /// Logarithm of the power that is left with the force up to 0, 1 … samples after; empty: nothing tells.
     std::vector<double> left() const {
-        if (rows_ < rows_per_column * columns) return {};
-        const VectorXd size = gram_.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-        MatrixXd scaled = size.asDiagonal() * MatrixXd(gram_.selfadjointView<Eigen::Lower>()) * size.asDiagonal();
+        if (sum_.kept() < samples_per_number * numbers) return {};
+        MatrixXd scaled = scaled_matrix(sum_.values()).values;
         scaled.diagonal().array() += ridge_of_unit;
         const MatrixXd factor = scaled.llt().matrixL();
         std::vector<double> out(most_late + 1);
         double sum = 0;
         for (std::size_t k = most_late + 1; k-- > 0;) {
-            sum += std::pow(factor(columns - 1, static_cast<Index>(2 * lags_before + 1 + k)), 2);
+            sum += std::pow(factor(numbers - 1, static_cast<Index>(2 * lags_before + 1 + k)), 2);
             out[k] = std::log(sum);
         }
         return out;
     }
 
   private:
-    static constexpr Index columns = 2 * lags_before + 2 + most_late;
-    static constexpr Index rows_per_column = 4;
+    static constexpr Index numbers = 2 * lags_before + 2 + most_late; // of the regression, the output last
+    static constexpr Index samples_per_number = 4;
 
-    void take(const Eigen::Ref<const MatrixXd>& rows) {
-        if (rows.cols() == 0) return;
-        gram_.selfadjointView<Eigen::Lower>().rankUpdate(rows);
-        rows_ += rows.cols();
-    }
-
-    MatrixXd gram_ = MatrixXd::Zero(columns, columns);
-    Index rows_ = 0;
+    gram_sum sum_{numbers};
 };
 
 /// The largest step down; 0: none that says that the force is late.
@@ -106,20 +93,14 @@ std::size_t step_down(const std::vector<double>& left) {
     return left[step - 1] - left[step] > std::log(judgement::answered_before) ? step : 0;
 }
 
-/// Does the force of every record act in hits?
-bool strikes(const record_set& set) {
-    return set.n_u == 1 && set.n_y > 0 &&
-           std::all_of(set.records.begin(), set.records.end(),
-                       [&](const record_data& record) { return acts_in_hits(from_rest(set, record, 0)); });
-}
-
 } // namespace
 
 std::size_t samples_late(const record_set& set) {
-    if (!strikes(set)) return 0;
+    if (set.n_u != 1) return 0;
     std::vector<future_fit> fits(std::min(set.n_y, outputs_asked));
     for (const record_data& record : set.records) {
         const std::vector<double> force = from_rest(set, record, 0);
+        if (!acts_in_hits(force)) return 0;
         const std::vector<std::size_t> samples = about_hits(force, most_rows / set.records.size());
         for (std::size_t i = 0; i < fits.size(); ++i)
             fits[i].add(force, from_rest(set, record, 1 + i * set.n_y / fits.size()), samples);

@@ -5,6 +5,8 @@
 // NUMERICS normal equations at unit diagonal with a ridge of 1e-10: coefficients that the record does not excite stay small
 #include "residue_fit.hpp"
 
+#include "gram_sum.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -16,7 +18,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr Index block = 256;
 constexpr double ridge = 1e-10;
 
 /// Modes in the model: poles and shapes.
@@ -41,20 +42,14 @@ MatrixXd gram_of(const modal_basis& basis, const record_set& set, const record_d
     const std::size_t n = basis.mu.size(), drives = set.n_u + (at_rest ? 0 : 1);
     const std::size_t near = 2 * static_cast<std::size_t>(beside) * set.n_u;
     const auto size = static_cast<Index>(2 * n * drives + set.channels() + near);
-    MatrixXd G = MatrixXd::Zero(size, size), X = MatrixXd::Zero(size, block);
+    gram_sum sum(size);
     std::vector<complex> z(n * drives);
     if (!at_rest) std::fill(z.begin() + static_cast<std::ptrdiff_t>(n * set.n_u), z.end(), complex(1));
-    Index filled = 0;
-    const auto fold = [&] {
-        if (filled > 0) G.selfadjointView<Eigen::Lower>().rankUpdate(X.leftCols(filled)); // 0: Eigen 3.4 divides by it
-        filled = 0;
-    };
     for (std::size_t t = 0; t < record.count; ++t) {
         const double* row = set.rows(record) + t * set.channels();
         if (std::any_of(row, row + set.n_u, [](double u) { return std::isnan(u); })) break;
         if (std::none_of(row + set.n_u, row + set.channels(), [](double y) { return std::isnan(y); })) {
-            auto x = X.col(filled++);
-            ++rows;
+            auto x = sum.next();
             for (std::size_t k = 0; k < z.size(); ++k) {
                 x[static_cast<Index>(2 * k)] = z[k].real();
                 x[static_cast<Index>(2 * k) + 1] = z[k].imag();
@@ -67,14 +62,15 @@ MatrixXd gram_of(const modal_basis& basis, const record_set& set, const record_d
                     const double* const force = set.rows(record) + (before ? t - lag : t + lag) * set.channels();
                     for (std::size_t j = 0; j < set.n_u; ++j) *other++ = there ? force[j] : 0;
                 }
-            if (filled == block) fold();
+            sum.keep();
         }
         for (std::size_t j = 0; j < drives; ++j)
             for (std::size_t k = 0; k < n; ++k)
                 z[j * n + k] = basis.mu[k] * z[j * n + k] + (j < set.n_u ? row[j] : 0.0);
     }
-    fold();
-    return G.selfadjointView<Eigen::Lower>();
+    sum.fold();
+    rows += static_cast<double>(sum.kept());
+    return sum.values();
 }
 
 /// What each unknown adds to output o, in the rows of the Gram matrix: modes of each drive, then D.

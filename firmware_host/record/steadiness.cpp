@@ -61,11 +61,18 @@ double time_covered(const std::vector<block_frequency>& over) {
     return (last - first) / (over.back().time - over.front().time);
 }
 
+/// How many blocks of equal weight would tell as much.
+double effective_number(const std::vector<block_frequency>& over) {
+    double total = 0, squares = 0;
+    for (const block_frequency& b : over) total += b.weight, squares += b.weight * b.weight;
+    return total * total / squares;
+}
+
 /// Covariance of the slopes where the scatter is larger in some blocks than in others, neighbours taken together.
 Matrix3d where_evidence_is(const std::vector<block_frequency>& over, double block_frequency::* level,
                            const Vector3d& mean, const Vector3d& slope, const Matrix3d& inverse) {
-    double total = 0, squares = 0, together = 0;
-    for (const block_frequency& b : over) total += b.weight, squares += b.weight * b.weight;
+    double total = 0, together = 0;
+    for (const block_frequency& b : over) total += b.weight;
     Matrix3d sum = Matrix3d::Zero();
     Vector3d group = Vector3d::Zero();
     for (const block_frequency& b : over) {
@@ -77,8 +84,8 @@ Matrix3d where_evidence_is(const std::vector<block_frequency>& over, double bloc
         group.setZero();
         together = 0;
     }
-    const double alike = total * total / squares; // blocks of equal weight
-    return inverse * sum * inverse * (alike / (alike - 3));
+    const double number = effective_number(over);
+    return inverse * sum * inverse * (number / (number - 3));
 }
 
 /// Weighted line over a power and time; changes from the quietest to the loudest tenth, and from begin to end.
@@ -86,14 +93,13 @@ slopes slopes_of(const std::vector<block_frequency>& over, double block_frequenc
     slopes out;
     std::vector<double> powers, times;
     Vector3d mean = Vector3d::Zero();
-    double total = 0, squares = 0;
+    double total = 0;
     for (const block_frequency& b : over) {
         powers.push_back(b.*level), times.push_back(b.time);
         mean += b.weight * Vector3d(0, b.*level, b.time);
         total += b.weight;
-        squares += b.weight * b.weight;
     }
-    if (!(total * total >= fewest_blocks * squares) || !(total > 0)) return out;
+    if (!(effective_number(over) >= fewest_blocks)) return out;
     mean /= total;
     Matrix3d N = Matrix3d::Zero();
     Vector3d h = Vector3d::Zero();
@@ -122,9 +128,7 @@ slopes slopes_of(const std::vector<block_frequency>& over, double block_frequenc
 /// The blocks without those that weigh most, so many of them as are a fifth of the effective number.
 std::vector<block_frequency> without_heaviest(std::vector<block_frequency> over) {
     std::sort(over.begin(), over.end(), [](const auto& a, const auto& b) { return a.weight < b.weight; });
-    double total = 0, squares = 0;
-    for (const block_frequency& b : over) total += b.weight, squares += b.weight * b.weight;
-    const double heavy = decisive * total * total / squares;
+    const double heavy = decisive * effective_number(over);
     over.resize(over.size() - std::min(over.size(), static_cast<std::size_t>(std::ceil(heavy))));
     std::sort(over.begin(), over.end(), [](const auto& a, const auto& b) { return a.time < b.time; });
     return over;
@@ -216,10 +220,9 @@ block_frequency corrected(const steady_search& s, const answered_record& record,
     Eigen::Matrix4d scaled = size.cwiseInverse().asDiagonal() * sums.N * size.cwiseInverse().asDiagonal();
     scaled.diagonal().array() += 1e-9;
     const Eigen::Matrix4d inverse = scaled.inverse();
-    const Eigen::Vector4d x = inverse * sums.h.cwiseQuotient(size);
+    const Eigen::Vector4d h = sums.h.cwiseQuotient(size), x = inverse * h;
     const double w = 2 * M_PI * s.modes[k]->frequency_hz;
-    const double after =
-        std::max(least_left * sums.power, sums.power - x.dot(sums.h.cwiseQuotient(size))) / sums.values;
+    const double after = std::max(least_left * sums.power, sums.power - x.dot(h)) / sums.values;
     return {x[0] / size[0] / w, power, motion / static_cast<double>(length), time,
             after > 0 ? size[0] * size[0] / inverse(0, 0) * w * w / after : 0};
 }
