@@ -2,8 +2,9 @@
 // PURPOSE  the modes that are in frequency responses
 // METHOD   poles of matrix fractions over degrees, weights of the lines and normalisations, of every set-up, are gathered by the
 //          agreement that method auto uses for records; those of the candidates are refined with the residues of all set-ups
-//          (modal_fit), and judged by the rule of records with the refined shape; the fit may strike out, never in. Shapes: the first singular vector of the residues at the references, the other entries
-//          by least squares on what each set-up has there
+//          (modal_fit), and judged by the rule of records with the refined shape; the fit strikes out what it does not know, and
+//          of measured responses believes what it knows well. Shapes: the first singular vector of the residues at the
+//          references, the other entries by least squares on what each set-up has there
 // REFERENCE Mevel, Basseville, Benveniste, Goursat (2002), several set-ups with references
 #include "response_modes.hpp"
 
@@ -11,6 +12,7 @@
 #include "error.hpp"
 #include "matrix_fraction.hpp"
 #include "record/request.hpp"
+#include "response_diagram.hpp"
 #include "result/hold.hpp"
 #include "result/judgement.hpp"
 
@@ -18,8 +20,6 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <memory>
-#include <okid/stabilization.h>
 #include <tuple>
 
 namespace okid_host {
@@ -30,7 +30,6 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr std::size_t middle_of_whole_band = 2;                   // among the runs of fit_matrix_fractions()
 constexpr int first_steps = 2, window_steps = 5, last_steps = 12; // of the poles
 constexpr std::ptrdiff_t lines_about = 2;                         // a frequency, to either side
 constexpr double neighbours = 0.02;                               // in frequency: poles that compete for one resonance
@@ -292,6 +291,16 @@ void choose_window(const std::vector<fitted_mode>& candidates, joint_responses& 
         from.window_s = 0;
 }
 
+/// Runs that scatter say little of a mode whose values and shape the fit of all responses knows.
+void believe_known(const fitted_mode& one, consensus_mode& mode) {
+    const double half_hz = mode.damping_ratio * mode.frequency_hz;
+    if (one.shape.shape.size() < judgement::fewest_outputs_known || mode.mpc < judgement::real_shape ||
+        one.shape.strength < judgement::known_strength || one.sigma.first > judgement::known_share * half_hz ||
+        one.sigma.second > judgement::known_share * mode.damping_ratio)
+        return;
+    mode.why.erase(std::remove(mode.why.begin(), mode.why.end(), "noise_shape"), mode.why.end());
+}
+
 /// The candidates at their refined values, with shapes and deviations; what turns out to be none is said.
 void refine_modes(joint_responses from, const std::vector<bool>& turned, response_modes& found) {
     auto& [modes, shapes, sigma, stable] = found;
@@ -310,6 +319,7 @@ void refine_modes(joint_responses from, const std::vector<bool>& turned, respons
         mode.damping_ratio = -one.pole.real() / std::abs(one.pole);
         mode.mpc = shape_collinearity(one.shape.shape, turned);
         judge_agreement(mode);
+        if (from.sample_s == 0) believe_known(one, mode); // measured responses
         std::tie(sigma.frequency_hz[one.at], sigma.damping_ratio[one.at]) = one.sigma;
         shapes[one.at] = std::move(one.shape);
     }
@@ -372,58 +382,6 @@ std::vector<consensus_run> runs_of(const joint_responses& from) {
             std::for_each(run.poles.begin(), run.poles.end(), seen);
             out.push_back(std::move(run));
         }
-    return out;
-}
-
-/// The poles of one order as the collector takes them.
-void add_model(const consensus_run& run, int order, int set_up, okid_stabilization_t* to, stabilization& out) {
-    std::vector<double> f, zeta, mpc, emac, re, im;
-    for (const run_pole& pole : run.poles) {
-        if (pole.order != order) continue;
-        f.push_back(pole.frequency_hz);
-        zeta.push_back(pole.damping_ratio);
-        mpc.push_back(pole.mpc);
-        emac.push_back(pole.emac);
-        for (const complex& entry : pole.shape) re.push_back(entry.real()), im.push_back(entry.imag());
-    }
-    okid_identified_t model{};
-    model.n_y = out.criteria.n_y;
-    model.n_z = order;
-    model.p = set_up;
-    model.mode_count = static_cast<std::int32_t>(f.size());
-    model.frequency_hz = f.data();
-    model.damping_ratio = zeta.data();
-    model.mpc = mpc.data();
-    model.emac = emac.data();
-    model.shape_re = re.data();
-    model.shape_im = im.data();
-    if (okid_stabilization_add(to, &model) == OKID_OK) out.models.emplace_back(set_up, order);
-}
-
-/// The poles over the whole band with the middle weight and the normalisation that keeps noise unstable, of every set-up: its number in the place of a horizon.
-stabilization diagram_of(const joint_responses& from, const std::vector<consensus_run>& runs) {
-    const std::size_t of_each = runs.size() / from.sets.size();
-    stabilization out;
-    out.criteria = okid_stabilization_defaults(static_cast<std::int32_t>(from.references.size()), 0, 1);
-    out.criteria.frequency = 0.01, out.criteria.damping = 0.05, out.criteria.mac = 0.98, out.criteria.share = 0.5;
-    std::vector<const consensus_run*> shown;
-    for (std::size_t j = 0; j < from.sets.size(); ++j) {
-        shown.push_back(&runs[j * of_each + middle_of_whole_band]);
-        out.criteria.max_models += static_cast<std::int32_t>(shown.back()->orders.size());
-        out.criteria.max_poles =
-            std::max(out.criteria.max_poles, static_cast<std::int32_t>(shown.back()->poles.size()));
-    }
-    const std::size_t bytes = okid_stabilization_memsize(&out.criteria);
-    const std::unique_ptr<std::byte[]> block(new std::byte[bytes]);
-    okid_stabilization_t* collector = nullptr;
-    if (bytes == 0 || okid_stabilization_create(&collector, &out.criteria, block.get(), bytes) != OKID_OK) return out;
-    for (std::size_t j = 0; j < shown.size(); ++j)
-        for (const int order : shown[j]->orders) add_model(*shown[j], order, static_cast<int>(j) + 1, collector, out);
-    okid_stabilized_t view{};
-    if (okid_stabilization_find(collector, &view) == OKID_OK) {
-        out.poles.assign(view.poles, view.poles + view.pole_count);
-        out.clusters.assign(view.clusters, view.clusters + view.cluster_count);
-    }
     return out;
 }
 

@@ -344,8 +344,8 @@ static std::optional<double> rate_of_rounded(const std::vector<double>& times) {
     if (uneven < 10) return {};
     double low = (duration - place) / steps, high = (duration + place) / steps, step = duration / steps;
     const double most = 1.001 * place + 4e-16 * std::abs(times.back());
-    while (spread_about(times, step) > most) { // it is convex in the slope
-        if (high - low < 1e-9 * place / steps) return {};
+    while (spread_about(times, step) > most) {                                    // it is convex in the slope
+        if (high - low < std::max(1e-9 * place / steps, 1e-15 * step)) return {}; // doubles know no finer
         const double a = low + (high - low) / 3, b = high - (high - low) / 3;
         if (spread_about(times, a) < spread_about(times, b))
             high = b;

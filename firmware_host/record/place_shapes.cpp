@@ -8,6 +8,8 @@
 
 #include "consensus/quantity.hpp"
 #include "result/drive_mass.hpp"
+#include "result/judgement.hpp"
+#include "result/mode_verdict.hpp"
 #include "roving.hpp"
 
 #include <algorithm>
@@ -74,18 +76,28 @@ class placer {
     }
 
   private:
-    /// Of the confident modes alone, so that a doubtful one takes nothing from them; then of the doubtful ones.
+    /// Of the doubtful modes beside all; then of the confident ones, beside those that are likely: what most runs found takes
+    /// its own motion, and noise takes nothing.
     place_residues residues_of(const std::vector<listed_mode>& modes, const record_options& options) const {
-        std::vector<listed_mode> all = modes;
-        for (listed_mode& mode : all) mode.in_model = true;
-        place_residues out = find_residues(all, options.hits, options.fs_hz, work_.set);
-        if (std::all_of(modes.begin(), modes.end(), [](const listed_mode& mode) { return mode.in_model; })) return out;
-        const place_residues confident = find_residues(modes, options.hits, options.fs_hz, work_.set);
+        const auto found = [&](const std::vector<listed_mode>& of) {
+            return find_residues(of, options.hits, options.fs_hz, work_.set);
+        };
+        std::vector<listed_mode> all = modes, likely = modes;
+        bool every = true;
+        for (std::size_t k = 0; k < modes.size(); ++k) {
+            const mode_verdict& verdict = work_.context.verdicts[k];
+            all[k].in_model = true;
+            likely[k].in_model |= verdict.found_in >= judgement::least_found_in && !is_tone(verdict.why);
+            every = every && likely[k].in_model;
+        }
+        place_residues out = found(all);
+        if (every) return out;
+        const place_residues alone = found(likely);
         Eigen::Index row = 0;
         for (std::size_t k = 0; k < modes.size(); ++k) {
-            if (!modes[k].in_model) continue;
-            out.b.row(static_cast<Eigen::Index>(k)) = confident.b.row(row);
-            out.std.row(static_cast<Eigen::Index>(k)) = confident.std.row(row++);
+            if (!likely[k].in_model) continue;
+            out.b.row(static_cast<Eigen::Index>(k)) = alone.b.row(row);
+            out.std.row(static_cast<Eigen::Index>(k)) = alone.std.row(row++);
         }
         return out;
     }

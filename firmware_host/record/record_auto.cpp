@@ -349,6 +349,15 @@ one_look picked_in(record_work seen, const record_options& options, const record
     return look_once(std::move(seen.set), seen.at_rest, options, about, seen.struck);
 }
 
+/// The look that is believed, as the result: frequencies that were picked are looked for in it.
+std::vector<listed_mode> take_look(one_look best, const record_options& options, record_work& work) {
+    if (!options.picks.empty()) best = picked_in(std::move(best.work), options, work);
+    if (best.listed.empty()) std::rethrow_exception(best.fault);
+    work = std::move(best.work);
+    work.struck = nullptr;
+    return best.listed;
+}
+
 /// Of records struck at different places: poles and shapes from all together, B and D from those of each place. What follows hits
 /// needs no input a place; with it modes are seen that die away soon, and the silence before. Who believes more modes counts.
 std::vector<listed_mode> find_struck(const record_options& options, const record_set& decays, record_work& work) {
@@ -359,34 +368,24 @@ std::vector<listed_mode> find_struck(const record_options& options, const record
     one_look best = look_once(free_decays(struck), false, unpicked(seen), work, &work.set),
              forced = look_once(work.set, true, unpicked(seen), work, nullptr); // nothing moved before
     if (forced.believed() > best.believed()) best = std::move(forced);
-    if (!options.picks.empty()) best = picked_in(std::move(best.work), seen, work);
-    if (best.listed.empty()) std::rethrow_exception(best.fault);
     const bool at_rest = work.at_rest;
-    work = std::move(best.work);
-    work.struck = nullptr;
-    refine_decays(decays, options, best.listed, work);
-    keep_numbers(options.modes, best.listed, work);
-    work.set = {};
-    work.set.n_y = struck.n_y;
-    make_modal_model(best.listed, options.fs_hz, work);
+    std::vector<listed_mode> listed = take_look(std::move(best), seen, work);
+    refine_decays(decays, options, listed, work);
     work.set = std::move(struck);
     work.at_rest = at_rest;
     if (options.detrend != "none") {
         remove_means(work.set);
         rest_forces(work.set);
     }
-    fit_places(best.listed, options.hits, options.fs_hz, work);
+    if (options.picks.empty()) doubt_scattered(listed, options.hits, options.fs_hz, work);
+    keep_numbers(options.modes, listed, work);
+    struck = std::exchange(work.set, {}); // the modes need no force
+    work.set.n_y = struck.n_y;
+    make_modal_model(listed, options.fs_hz, work);
+    work.set = std::move(struck);
+    fit_places(listed, options.hits, options.fs_hz, work);
     remark_low_fit(*work.context.simulation_percent, true, work.context);
-    return best.listed;
-}
-
-/// The look that is believed, as the result: frequencies that were picked are looked for in it.
-std::vector<listed_mode> take_look(one_look best, const record_options& options, record_work& work) {
-    if (!options.picks.empty()) best = picked_in(std::move(best.work), options, work);
-    if (best.listed.empty()) std::rethrow_exception(best.fault);
-    work = std::move(best.work);
-    work.struck = nullptr;
-    return best.listed;
+    return listed;
 }
 
 /// Without a force: a train drives the structure at frequencies of its own, what follows it is a free decay, as after a release.

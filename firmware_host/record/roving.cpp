@@ -102,6 +102,22 @@ std::string contradiction_text(const record_set& set, const std::vector<residue_
         text, 100 * std::min(worst, 1.0), 100 * own);
 }
 
+/// What one B and D cannot explain of the records of each place, or of all.
+std::vector<std::string> contradictions(const std::vector<listed_mode>& modes, const std::vector<int>& hits,
+                                        double fs_hz, const record_work& work) {
+    std::vector<std::string> out;
+    if (work.set.records.size() < 2 || work.set.n_u == 0) return out;
+    const auto sums = sum_residues(modes, fs_hz, work.set, work.at_rest || are_blows(work.set));
+    for (const int place : hits.empty() ? std::vector<int>{0} : hit_places(hits)) {
+        std::vector<std::size_t> records;
+        for (std::size_t r = 0; r < sums.size(); ++r)
+            if (hits.empty() || hits[r] == place) records.push_back(r);
+        std::string text = records.size() < 2 ? "" : contradiction_text(work.set, sums, records);
+        if (!text.empty()) out.push_back(std::move(text));
+    }
+    return out;
+}
+
 } // namespace
 
 bool are_blows(const record_set& set) {
@@ -240,6 +256,18 @@ place_residues find_residues(const std::vector<listed_mode>& modes, const std::v
     return out;
 }
 
+void doubt_scattered(std::vector<listed_mode>& modes, const std::vector<int>& hits, double fs_hz, record_work& work) {
+    if (!contradictions(modes, hits, fs_hz, work).empty()) return; // struck elsewhere than is said: no noise
+    const place_residues found = find_residues(modes, hits, fs_hz, work.set);
+    Eigen::Index row = 0;
+    for (std::size_t k = 0; k < modes.size(); ++k) {
+        if (!modes[k].in_model) continue;
+        if (found.b.row(row).norm() < judgement::least_strength * found.std.row(row).norm())
+            doubt("noise_shape", work.context.verdicts[k], modes[k]);
+        ++row;
+    }
+}
+
 void check_hits(const record_set& set, const std::vector<int>& hits) {
     if (!hits.empty() && hits.size() != set.records.size())
         throw failure(exit_usage, fmt::format("--hit-dofs: found {} numbers for {} records, expected one for each",
@@ -262,15 +290,8 @@ void remark_contradiction(const std::vector<listed_mode>& modes, const std::vect
                           record_work& work) {
     if (const std::string text = moved_outputs_text(modes, work.context.sigma, fs_hz, work.set); !text.empty())
         work.context.warnings.emplace_back("records_contradict", text);
-    if (work.set.records.size() < 2 || work.set.n_u == 0) return;
-    const auto sums = sum_residues(modes, fs_hz, work.set, work.at_rest || are_blows(work.set));
-    for (const int place : hits.empty() ? std::vector<int>{0} : hit_places(hits)) {
-        std::vector<std::size_t> records;
-        for (std::size_t r = 0; r < sums.size(); ++r)
-            if (hits.empty() || hits[r] == place) records.push_back(r);
-        const std::string text = records.size() < 2 ? "" : contradiction_text(work.set, sums, records);
-        if (!text.empty()) work.context.warnings.emplace_back("records_contradict", text);
-    }
+    for (const std::string& text : contradictions(modes, hits, fs_hz, work))
+        work.context.warnings.emplace_back("records_contradict", text);
 }
 
 } // namespace okid_host

@@ -59,6 +59,12 @@ constexpr double nearly_all =
     0.9; ///< of the runs that vote: where so many see both, two are two (pairs of tests/kinds)
 constexpr double same_residues = 0.9; ///< MAC of the residues of two poles that are one mode, of responses
 
+// Of measured responses, a mode that the fit knows though runs scatter.
+constexpr std::size_t fewest_outputs_known = 3; ///< with fewer, two points in phase are chance
+constexpr double real_shape = 0.95;             ///< MPC
+constexpr double known_strength = 5;            ///< of its residues over their noise
+constexpr double known_share = 0.1;             ///< of the half-width: deviations of f and of damping
+
 // A line: a vibration that a machine keeps up, and no resonance.
 constexpr double steady = 0.25;     ///< spread over mean of an amplitude; 0.52 for noise in a narrow band (Rice 1945)
 constexpr double of_chance = 0.52;  ///< … of a vibration under chance forces

@@ -173,9 +173,10 @@ def _stand_out(file: File, noise_of: Real) -> list[int]:
     return out
 
 
-def make(kind: str, name: str, seed: int, repeat: int = 0, drift: float = 3e-4) -> File:
-    """One file. @param repeat  other noise, other forces, the same structure and points."""
+def make(kind: str, name: str, seed: int, repeat: int = 0, drift: float = 3e-4, damping: float = 1) -> File:
+    """One file. @param repeat  other noise, other forces, the same structure, points. @param damping  times as much"""
     of = structure(name, seed)
+    of.zeta *= damping
     r = np.random.default_rng([seed, KINDS.index(kind), STRUCTURES.index(name), 1])  # the test
     n = np.random.default_rng([seed, KINDS.index(kind), STRUCTURES.index(name), 2, repeat])  # what chance does
     points = list(range(len(of.phi)))

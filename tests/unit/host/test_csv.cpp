@@ -221,9 +221,11 @@ void rounded_stamps() {
     for (const int row : {40, 150, 299}) refused(stamped("time_s", 1024, 3, 400, row), "missing");
     refused(stamped("time_s", 1024, 3, 90), "evenly spaced"); // too few to tell
     refused(stamped("time_s", 100, 2, 600, 300), "missing");  // as 99.83 Hz would be, rounded
-    std::string jitter = "time_s,a,b\n";
-    for (int i = 0; i < 1000; ++i) jitter += std::to_string(i / 1000.0 + 3e-4 * (i * i % 17 / 17.0)) + ",1,2\n";
-    refused(jitter, "evenly spaced");
+    for (const double fs : {1000.0, 100.0}) { // a search for the rate must end where doubles tell none apart
+        std::string jitter = "time_s,a,b\n";
+        for (int i = 0; i < 6000; ++i) jitter += std::to_string((i + 0.3 * (i * i % 17 / 17.0)) / fs) + ",1,2\n";
+        refused(jitter, "evenly spaced");
+    }
 }
 
 void refusals() {
