@@ -2,7 +2,8 @@
 // PURPOSE  where the modes of auto are now, between two decisions which they are
 // METHOD   the filters of consensus/levels.hpp sample by sample, an accumulator for each rate. The models that carried the modes
 //          when they were decided are made again; a mode moves by the share of the move of its carrier that is not the carrier's
-//          own noise, and keeps what the runs agreed on
+//          own noise, and keeps what the runs agreed on. Where the result rests on a part of the rows, as on free decays, it stays:
+//          the sums hold all of them
 #include "followed_modes.hpp"
 
 #include "consensus/consensus_runs.hpp"
@@ -120,6 +121,10 @@ void followed_modes::begin(const record_result& found) {
     units_.clear();
     for (const double spread : found.scale) units_.push_back(1 / spread);
     for (const owned_sums& each : sums_) okid_accumulator_set_units(each.sums, units_.data(), nullptr);
+    const remarks& said = found.context.warnings;
+    const bool of_part = std::any_of(said.begin(), said.end(), [](const auto& one) {
+        return one.first == "free_decays" || one.first == "force_window";
+    });
     for (std::size_t i = 0; i < found.carriers.size(); ++i) {
         const mode_carrier& by = found.carriers[i];
         if (by.level < 0) continue;
@@ -135,8 +140,8 @@ void followed_modes::begin(const record_result& found) {
             at->config.detrend = OKID_DETREND_MEAN;
         }
         const std::optional<deviations>& sigma = found.context.sigma;
-        at->modes.push_back({i, share_of(sigma ? sigma->frequency_hz[i] : NAN, by.frequency_std_hz),
-                             share_of(sigma ? sigma->damping_ratio[i] : NAN, by.damping_std)});
+        at->modes.push_back({i, of_part ? 0 : share_of(sigma ? sigma->frequency_hz[i] : NAN, by.frequency_std_hz),
+                             of_part ? 0 : share_of(sigma ? sigma->damping_ratio[i] : NAN, by.damping_std)});
         at->wanted.push_back({by.frequency_hz, by.damping_ratio, by.shape});
     }
     for (group& one : groups_) one.then = now(one);

@@ -101,8 +101,8 @@ void describe_modes(const std::vector<listed_pair>& found, const std::vector<dou
         throw failure(
             exit_no_model,
             "no model: no run of any method was possible: too few samples follow one another without a missing or "
-            "screened one between them. Record longer, fix the gaps, set the sensors to a range that they do not "
-            "leave, or look at one method with --method n4sid-cva");
+            "screened one, or a force has too few frequencies, as a sine. Record longer, fix the gaps, set sensors to "
+            "a range that they do not leave, or see what --method n4sid-cva says");
     std::string seen;
     for (const auto& [mode, carried] : found)
         if (mode.agreement > judgement::worth_listing)

@@ -83,6 +83,23 @@ def test_a_bad_record_costs_itself_and_silence_costs_its_group(tmp_path: Path, c
     assert sum(bool(done.result["modes"]) for done in out.done.values()) == SMALL.records - 2
 
 
+def test_missing_numbers_are_counted_and_a_record_of_none_is_left_out(tmp_path: Path, client: Any) -> None:
+    spec = default(tmp_path)
+    paths = sorted((tmp_path / "records").iterdir())[:3]
+    first, empty, dead = (np.load(path).astype(float) * np.array(spec.channels.scale) for path in paths)
+    first[100:140, 2] = first[130:150, 1] = np.nan
+    empty[:], dead[:, 3] = np.nan, np.nan  # a channel without a number costs no rows
+    for path, samples in zip(paths, (first, empty, dead), strict=True):
+        np.save(path, samples)
+    out = run_campaign(spec, client)
+    assert [(one.name, one.reason) for one in out.skipped] == [
+        (f"records/{paths[1].name}", "holds no number in any row")
+    ]
+    counted = {one["name"]: one["missing"] for done in out.done.values() for one in done.records}
+    assert [counted.pop(f"records/{path.name}") for path in (paths[0], paths[2])] == [50, 0]
+    assert set(counted.values()) == {0}
+
+
 def test_codes_at_full_scale_are_left_out_when_asked(tmp_path: Path, client: Any) -> None:
     spec = default(tmp_path, {"fs_hz": 'saturated = "missing"\nfs_hz'})
     path = sorted((tmp_path / "records").iterdir())[0]

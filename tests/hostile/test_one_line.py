@@ -266,6 +266,16 @@ def test_messages_name_the_cause(
     assert done.returncode == code and len(done.stderr.splitlines()) == 1 and words in done.stderr, done
 
 
+def test_a_force_of_one_frequency(tmp_path: Path) -> None:
+    """All samples are there, and it said that too few of them were."""
+    dice = np.random.default_rng(1)
+    force = np.sin(2 * np.pi * 5 * np.arange(6000) / 100)
+    rows = np.column_stack([force, np.roll(force, 3) + 0.01 * dice.standard_normal(6000)])
+    np.savetxt(tmp_path / "x.csv", rows, delimiter=",", header="# fs_hz: 100\nu,y", comments="")
+    done = measured("identify", tmp_path / "x.csv", "--inputs", "u", "--outputs", "y", within_s=300)
+    assert done.returncode == 3 and "a force has too few frequencies" in done.stderr, done
+
+
 @pytest.mark.parametrize("part", ["re", "im"])
 def test_frequency_responses_of_one_part(tmp_path: Path, part: str) -> None:
     """Real parts alone were taken for responses."""

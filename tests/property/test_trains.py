@@ -109,3 +109,16 @@ def test_numbers_of_modes_are_those_of_the_table(tmp_path: Path) -> None:
         for block in np.array_split(y, 7):
             session.feed(block)
         assert [m.frequency_hz for m in session.identify().modes] == [m["frequency_hz"] for m in every["modes"]]
+
+
+def test_a_stream_keeps_what_the_decays_tell_until_it_decides_again() -> None:
+    """Its sums hold the trains, too, and would move the modes by many deviations."""
+    rows = trains(1)
+    stream = okid.Session(0, len(SENSORS), fs=FS)
+    stream.feed(rows[:16000])
+    decided = stream.modes()
+    assert "free_decays" in [one.code for one in stream.identify().warnings]
+    for first in (16000, 16800):
+        stream.feed(rows[first : first + 800])
+        for then, now in zip(decided, stream.modes(), strict=True):
+            assert (now.frequency_hz, now.damping_ratio) == (then.frequency_hz, then.damping_ratio)

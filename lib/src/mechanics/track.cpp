@@ -35,6 +35,7 @@ namespace {
 
 constexpr double alone = 1;        // the cost of a mode without a track
 constexpr double remembered = 0.1; // weight of the newest shape in the mean, at least
+constexpr int missed = 10;         // part of the updates after which a track ends: it is not coming back
 constexpr double by_memory = 0.35; // weight of the mean beside the shape last seen: what veers follows the latter
 
 size_t lay_out(okid_tracks& s, okid::arena& memory) {
@@ -188,16 +189,21 @@ void see(okid_tracks& s, int k, const mode_view& modes, int mode) {
     if (s.close[k] == 0 || track.hits == 1) remember(s, k);
 }
 
+/// Of track k from track j, which was lost.
+double distance_of_track(const okid_tracks& s, int k, int j) {
+    const auto frequency = static_cast<okid_real_t>(s.track[k].frequency_hz);
+    const mode_view one{&frequency, nullptr, s.shape_re + column_of(s, k), s.shape_im + column_of(s, k)};
+    return distance(s, one, 0, j, true);
+}
+
 /// The lost track that candidate k, seen for `born` updates, goes on with: the nearest of those not seen since it appeared
 /// (then they may have shared an update, of old and new samples mixed).
 int lost_track(const okid_tracks& s, int k) {
-    const auto frequency = static_cast<okid_real_t>(s.track[k].frequency_hz);
-    const mode_view one{&frequency, nullptr, s.shape_re + column_of(s, k), s.shape_im + column_of(s, k)};
     int best = -1;
     double least = alone;
     for (int j = 0; j < s.count; ++j) {
         if (s.track[j].number == 0 || s.track[j].misses < s.config.born - 1) continue;
-        const double d = distance(s, one, 0, j, true);
+        const double d = distance_of_track(s, k, j);
         if (d < least) least = d, best = j;
     }
     return best;
@@ -236,6 +242,29 @@ void give_birth(okid_tracks& s, int modes) {
         if (lost < 0) continue;
         s.track[k].hits += s.track[lost].hits;
         remove(s, lost);
+    }
+}
+
+/// A mode that moved stood beside itself while the models held samples from before and behind: the younger of two has a number
+/// of its own when the older one is not seen any more, and takes its number.
+void marry(okid_tracks& s) {
+    for (int j = s.count - 1; j >= 0; --j) {
+        const okid_track_t old = s.track[j];
+        if (old.number == 0 || old.misses != std::max(s.config.born, s.config.dies / missed)) continue;
+        int best = -1;
+        double least = alone;
+        for (int k = 0; k < s.count; ++k) {
+            const okid_track_t& one = s.track[k];
+            if (one.number <= old.number || one.misses > 0) continue;
+            if (one.hits - old.misses > std::min(old.hits, s.config.dies))
+                continue; // stood beside it for long: another mode
+            const double d = distance_of_track(s, k, j);
+            if (d < least) least = d, best = k;
+        }
+        if (best < 0) continue;
+        s.track[best].number = old.number;
+        s.track[best].hits += old.hits;
+        remove(s, j);
     }
 }
 
@@ -293,6 +322,7 @@ okid_status_t okid_track_update(okid_tracks_t* self, int32_t count, const okid_r
         see(s, k, modes, m);
     }
     give_birth(s, count);
+    marry(s);
     std::fill(number, number + count, 0);
     for (int k = 0; k < s.count; ++k)
         if (s.mode[k] >= 0) number[s.mode[k]] = s.track[k].number;

@@ -196,6 +196,40 @@ static void a_jump_is_followed_by_the_shape(void) {
 }
 
 // A change that is known of: no waiting for three hits, and what stood between is nothing.
+/// So many updates of three modes with a fourth at 8 Hz, and so many without the one at 10 Hz. @return number of the one at 8 Hz
+static int stood_beside(int both, int alone, int kind) {
+    settle();
+    for (int k = 0; k < both; ++k) {
+        three_modes(1);
+        put(8, kind, 0.5);
+        update();
+        expect(1, 2, 3);
+        TEST_ASSERT_EQUAL_INT(k < 2 ? 0 : 4, number[3]);
+    }
+    for (int k = 0; k < alone; ++k) {
+        put(8, kind, 0.5);
+        put(20, 1, 1);
+        put(40, 2, 2);
+        update();
+        TEST_ASSERT_EQUAL_INT(2, number[1]);
+        TEST_ASSERT_EQUAL_INT(3, number[2]);
+    }
+    return number[0];
+}
+
+static void a_mode_that_stood_beside_itself_keeps_its_number(void) {
+    TEST_ASSERT_EQUAL_INT(4, stood_beside(40, 9, 0)); // it may come back
+    setUp();
+    TEST_ASSERT_EQUAL_INT(1, stood_beside(40, 10, 0));
+    put(8, 0, 0.5);
+    update();
+    TEST_ASSERT_EQUAL_INT(1, number[0]);
+    setUp();
+    TEST_ASSERT_EQUAL_INT(4, stood_beside(40, 60, 1)); // of another shape
+    setUp();
+    TEST_ASSERT_EQUAL_INT(4, stood_beside(120, 60, 0)); // a mode of its own, for as long as tracks live
+}
+
 static void an_announced_jump(void) {
     settle();
     for (int k = 0; k < 2; ++k) { // of samples from before and after
@@ -297,6 +331,7 @@ int main(void) {
     RUN_TEST(close_modes_that_swap_order_keep_their_identity);
     RUN_TEST(the_assignment_is_the_best);
     RUN_TEST(a_jump_is_followed_by_the_shape);
+    RUN_TEST(a_mode_that_stood_beside_itself_keeps_its_number);
     RUN_TEST(an_announced_jump);
     RUN_TEST(as_good_as_every_permutation);
     RUN_TEST(a_full_house_takes_no_more);

@@ -144,10 +144,16 @@ def _of_file(spec: CampaignSpec, kind: str, path: Path) -> tuple[NDArray[Any], f
 
 
 def _as_codes(spec: CampaignSpec, name: str, samples: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
-    """The samples as the accumulator takes them; which are missing, None = none. Auto takes them as they are."""
+    """The samples as the accumulator takes them; which are missing, None = none. Auto takes them as they are, and does
+    without a channel that has no number."""
     codes = spec.channels.codes
     if spec.identification.method == "auto":
-        return samples, None
+        known = np.isfinite(samples)
+        alive = known.any(axis=0)
+        if not np.any(alive):
+            raise InputError(f"{name}: holds no number in any row")
+        absent = ~np.all(known[:, alive], axis=1)
+        return samples, absent if np.any(absent) else None
     if samples.dtype.kind == "f":
         absent = ~np.all(np.isfinite(samples), axis=1)
         missing = absent if np.any(absent) else None
