@@ -4,6 +4,8 @@
 //          its number in the place of a horizon
 #include "response_diagram.hpp"
 
+#include "record/record_work.hpp"
+
 #include <algorithm>
 #include <complex>
 #include <cstddef>
@@ -17,26 +19,22 @@ constexpr std::size_t middle_of_whole_band = 2; // among the runs of fit_matrix_
 
 /// The poles of one order as the collector takes them.
 void add_model(const consensus_run& run, int order, int set_up, okid_stabilization_t* to, stabilization& out) {
-    std::vector<double> f, zeta, mpc, emac, re, im;
+    refined_arrays poles;
     for (const run_pole& pole : run.poles) {
         if (pole.order != order) continue;
-        f.push_back(pole.frequency_hz);
-        zeta.push_back(pole.damping_ratio);
-        mpc.push_back(pole.mpc);
-        emac.push_back(pole.emac);
-        for (const std::complex<double>& entry : pole.shape) re.push_back(entry.real()), im.push_back(entry.imag());
+        poles.frequency.push_back(pole.frequency_hz);
+        poles.damping.push_back(pole.damping_ratio);
+        poles.mpc.push_back(pole.mpc);
+        poles.emac.push_back(pole.emac);
+        for (const std::complex<double>& entry : pole.shape)
+            poles.shape_re.push_back(entry.real()), poles.shape_im.push_back(entry.imag());
     }
     okid_identified_t model{};
     model.n_y = out.criteria.n_y;
     model.n_z = order;
     model.p = set_up;
-    model.mode_count = static_cast<std::int32_t>(f.size());
-    model.frequency_hz = f.data();
-    model.damping_ratio = zeta.data();
-    model.mpc = mpc.data();
-    model.emac = emac.data();
-    model.shape_re = re.data();
-    model.shape_im = im.data();
+    model.mode_count = static_cast<std::int32_t>(poles.frequency.size());
+    poles.show_modes(model);
     if (okid_stabilization_add(to, &model) == OKID_OK) out.models.emplace_back(set_up, order);
 }
 

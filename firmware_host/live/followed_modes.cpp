@@ -121,10 +121,7 @@ void followed_modes::begin(const record_result& found) {
     units_.clear();
     for (const double spread : found.scale) units_.push_back(1 / spread);
     for (const owned_sums& each : sums_) okid_accumulator_set_units(each.sums, units_.data(), nullptr);
-    const remarks& said = found.context.warnings;
-    const bool of_part = std::any_of(said.begin(), said.end(), [](const auto& one) {
-        return one.first == "free_decays" || one.first == "force_window";
-    });
+    of_part_ = has_remark(found.context.warnings, "free_decays") || has_remark(found.context.warnings, "force_window");
     for (std::size_t i = 0; i < found.carriers.size(); ++i) {
         const mode_carrier& by = found.carriers[i];
         if (by.level < 0) continue;
@@ -140,14 +137,16 @@ void followed_modes::begin(const record_result& found) {
             at->config.detrend = OKID_DETREND_MEAN;
         }
         const std::optional<deviations>& sigma = found.context.sigma;
-        at->modes.push_back({i, of_part ? 0 : share_of(sigma ? sigma->frequency_hz[i] : NAN, by.frequency_std_hz),
-                             of_part ? 0 : share_of(sigma ? sigma->damping_ratio[i] : NAN, by.damping_std)});
+        at->modes.push_back({i, share_of(sigma ? sigma->frequency_hz[i] : NAN, by.frequency_std_hz),
+                             share_of(sigma ? sigma->damping_ratio[i] : NAN, by.damping_std)});
         at->wanted.push_back({by.frequency_hz, by.damping_ratio, by.shape});
     }
+    if (of_part_) return;
     for (group& one : groups_) one.then = now(one);
 }
 
 void followed_modes::follow(double kept, kept_model& to, std::optional<deviations>& sigma) {
+    if (of_part_) return;
     double *f = to.own(to.view().frequency_hz), *zeta = to.own(to.view().damping_ratio);
     for (const group& one : groups_) {
         const auto found = now(one);

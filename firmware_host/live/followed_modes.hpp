@@ -58,6 +58,7 @@ class followed_modes {
     std::size_t m_;
     rate_chain chain_;
     std::vector<owned_sums> sums_; ///< of each rate
+    bool of_part_ = false;         ///< the modes rest on a part of the rows, the sums hold all: they stay
     std::vector<double> missing_, units_;
     std::vector<group> groups_;
 };

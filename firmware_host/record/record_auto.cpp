@@ -371,18 +371,17 @@ std::vector<listed_mode> find_struck(const record_options& options, const record
     const bool at_rest = work.at_rest;
     std::vector<listed_mode> listed = take_look(std::move(best), seen, work);
     refine_decays(decays, options, listed, work);
-    work.set = std::move(struck);
-    work.at_rest = at_rest;
     if (options.detrend != "none") {
-        remove_means(work.set);
-        rest_forces(work.set);
+        remove_means(struck);
+        rest_forces(struck);
     }
-    if (options.picks.empty()) doubt_scattered(listed, options.hits, options.fs_hz, work);
+    if (options.picks.empty()) doubt_scattered(options.hits, options.fs_hz, struck, listed, work.context.verdicts);
     keep_numbers(options.modes, listed, work);
-    struck = std::exchange(work.set, {}); // the modes need no force
+    work.set = {};
     work.set.n_y = struck.n_y;
     make_modal_model(listed, options.fs_hz, work);
     work.set = std::move(struck);
+    work.at_rest = at_rest;
     fit_places(listed, options.hits, options.fs_hz, work);
     remark_low_fit(*work.context.simulation_percent, true, work.context);
     return listed;

@@ -104,15 +104,15 @@ std::string contradiction_text(const record_set& set, const std::vector<residue_
 
 /// What one B and D cannot explain of the records of each place, or of all.
 std::vector<std::string> contradictions(const std::vector<listed_mode>& modes, const std::vector<int>& hits,
-                                        double fs_hz, const record_work& work) {
+                                        double fs_hz, const record_set& set, bool at_rest) {
     std::vector<std::string> out;
-    if (work.set.records.size() < 2 || work.set.n_u == 0) return out;
-    const auto sums = sum_residues(modes, fs_hz, work.set, work.at_rest || are_blows(work.set));
+    if (set.records.size() < 2 || set.n_u == 0) return out;
+    const auto sums = sum_residues(modes, fs_hz, set, at_rest || are_blows(set));
     for (const int place : hits.empty() ? std::vector<int>{0} : hit_places(hits)) {
         std::vector<std::size_t> records;
         for (std::size_t r = 0; r < sums.size(); ++r)
             if (hits.empty() || hits[r] == place) records.push_back(r);
-        std::string text = records.size() < 2 ? "" : contradiction_text(work.set, sums, records);
+        std::string text = records.size() < 2 ? "" : contradiction_text(set, sums, records);
         if (!text.empty()) out.push_back(std::move(text));
     }
     return out;
@@ -256,14 +256,15 @@ place_residues find_residues(const std::vector<listed_mode>& modes, const std::v
     return out;
 }
 
-void doubt_scattered(std::vector<listed_mode>& modes, const std::vector<int>& hits, double fs_hz, record_work& work) {
-    if (!contradictions(modes, hits, fs_hz, work).empty()) return; // struck elsewhere than is said: no noise
-    const place_residues found = find_residues(modes, hits, fs_hz, work.set);
+void doubt_scattered(const std::vector<int>& hits, double fs_hz, const record_set& blows,
+                     std::vector<listed_mode>& modes, std::vector<mode_verdict>& verdicts) {
+    if (!contradictions(modes, hits, fs_hz, blows, true).empty()) return; // struck elsewhere than is said: no noise
+    const place_residues found = find_residues(modes, hits, fs_hz, blows);
     Eigen::Index row = 0;
     for (std::size_t k = 0; k < modes.size(); ++k) {
         if (!modes[k].in_model) continue;
         if (found.b.row(row).norm() < judgement::least_strength * found.std.row(row).norm())
-            doubt("noise_shape", work.context.verdicts[k], modes[k]);
+            doubt("noise_shape", verdicts[k], modes[k]);
         ++row;
     }
 }
@@ -290,7 +291,7 @@ void remark_contradiction(const std::vector<listed_mode>& modes, const std::vect
                           record_work& work) {
     if (const std::string text = moved_outputs_text(modes, work.context.sigma, fs_hz, work.set); !text.empty())
         work.context.warnings.emplace_back("records_contradict", text);
-    for (const std::string& text : contradictions(modes, hits, fs_hz, work))
+    for (const std::string& text : contradictions(modes, hits, fs_hz, work.set, work.at_rest))
         work.context.warnings.emplace_back("records_contradict", text);
 }
 

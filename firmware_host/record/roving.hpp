@@ -43,7 +43,8 @@ place_residues find_residues(const std::vector<listed_mode>& modes, const std::v
 
 /// A mode is doubtful (`noise_shape`) whose residues over all places are below twice what hits of one place scatter: a hum, say,
 /// is in every hit, with another phase. None is where records contradict each other.
-void doubt_scattered(std::vector<listed_mode>& modes, const std::vector<int>& hits, double fs_hz, record_work& work);
+void doubt_scattered(const std::vector<int>& hits, double fs_hz, const record_set& blows,
+                     std::vector<listed_mode>& modes, std::vector<mode_verdict>& verdicts);
 
 /// The modes of a model, those of little EMAC not in it.
 std::vector<listed_mode> modes_of(const okid_identified_t& model);

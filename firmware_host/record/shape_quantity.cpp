@@ -84,8 +84,7 @@ void shapes_in_one_quantity(const std::vector<int>& sensing, kept_model& model, 
 }
 
 void shapes_without_delays(kept_model& model, result_context& context) {
-    const auto mixed = [](const auto& warning) { return warning.first == "mixed_quantities"; };
-    if (context.placed || std::any_of(context.warnings.begin(), context.warnings.end(), mixed)) return;
+    if (context.placed || has_remark(context.warnings, "mixed_quantities")) return;
     const std::vector<late_output> late = late_outputs(confident_shapes(model.view(), context));
     if (late.empty()) return;
     std::vector<double> seconds(context.outputs.size());

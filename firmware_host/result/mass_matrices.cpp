@@ -277,6 +277,10 @@ void take_units(const std::vector<std::string>& units, mass_plan& plan, remarks&
     }
 }
 
+bool has_remark(const remarks& said, const char* code) {
+    return std::any_of(said.begin(), said.end(), [&](const auto& each) { return each.first == code; });
+}
+
 mass_matrices find_mass_matrices(const okid_identified_t& model, const mass_plan& plan, remarks& said) {
     const attempt tried = try_plan(model, plan);
     if (tried.status < 0) throw_no_matrices(tried, model, plan);
@@ -286,9 +290,8 @@ mass_matrices find_mass_matrices(const okid_identified_t& model, const mass_plan
     find_motion_at_forces(model, plan, found);
     const remarks notes = mass_remarks(found);
     said.insert(said.end(), notes.begin(), notes.end());
-    const bool misread =
-        std::any_of(said.begin(), said.end(), [](const auto& each) { return each.first == "code_jumps"; });
-    if (!(found.notes & doubts) || misread) return found; // misread numbers are the cause, and no guess finds it
+    if (!(found.notes & doubts)) return found;
+    if (has_remark(said, "code_jumps")) return found; // misread numbers are the cause, and no guess finds it
     const std::string cause = likely_cause(model, plan);
     if (!cause.empty()) said.emplace_back("mkr_likely_cause", fmt::format("every check passes with {}", cause));
     return found;

@@ -31,6 +31,7 @@ struct mass_plan {
 };
 
 using remarks = std::vector<std::pair<std::string, std::string>>; ///< (code, text)
+bool has_remark(const remarks& said, const char* code);
 
 /// A mode that went into the matrices.
 struct mass_mode {

@@ -369,10 +369,7 @@ std::vector<std::pair<std::string, std::string>> result_warnings(const okid_iden
     const std::string without = confident_modes(model, context, [](double, double f_std, double, double zeta_std) {
         return !std::isfinite(f_std) || !std::isfinite(zeta_std);
     });
-    const auto said = [&](const char* code) {
-        return std::any_of(out.begin(), out.end(), [&](const auto& one) { return one.first == code; });
-    };
-    if (!without.empty() && !said("no_deviation") && context.method != "poser")
+    if (!without.empty() && !has_remark(out, "no_deviation") && context.method != "poser")
         out.emplace_back(
             "no_deviation",
             fmt::format("no ± for {}: with some block of the record left out, the model does not hold it. {}", without,
@@ -382,7 +379,7 @@ std::vector<std::pair<std::string, std::string>> result_warnings(const okid_iden
     const std::string wide = confident_modes(model, context, [](double f, double f_std, double zeta, double zeta_std) {
         return f_std > judgement::widest_frequency * f || zeta_std > judgement::wide_damping * zeta;
     });
-    if (!wide.empty() && judged_by_agreement(context) && !said("wide_sigma"))
+    if (!wide.empty() && judged_by_agreement(context) && !has_remark(out, "wide_sigma"))
         out.emplace_back("wide_sigma", fmt::format("one standard deviation is as large as the damping, or {:.0f} % of "
                                                    "the frequency, at {}: with some block of the record left out, the "
                                                    "model has it elsewhere",

@@ -2,8 +2,8 @@
 /// @file track.h
 /// Modes followed from update to update: which mode of this model is which mode of the one before. A track has a number
 /// that is never given to another; a mode that is absent for a while keeps it, and so does one that jumps (a structure that
-/// was changed), as far as its shape is known again. Where a window holds samples from before and behind, both stand for a
-/// while: the younger takes the number when the older one was missed `dies`/10 times.
+/// was changed), as far as its shape is known again. Where a model holds samples from before and after the jump, the mode
+/// stands at both places for a while; the new one takes the number when the old one was missed `dies`/10 times.
 #ifndef OKID_TRACK_H
 #define OKID_TRACK_H
 

@@ -232,21 +232,28 @@ int holder(const okid_tracks& s, int mode) {
     return static_cast<int>(std::find(s.mode, s.mode + s.count, mode) - s.mode);
 }
 
+/// Track k goes on with the number of track j, which ends.
+void take_over(okid_tracks& s, int k, int j) {
+    s.track[k].number = s.track[j].number;
+    s.track[k].hits += s.track[j].hits;
+    remove(s, j);
+}
+
 /// Candidates seen often enough become tracks, in the order of their frequencies, or go on with one.
 void give_birth(okid_tracks& s, int modes) {
     for (int mode = 0; mode < modes; ++mode) {
         const int k = holder(s, mode);
         if (k == s.count || s.track[k].number != 0 || s.track[k].hits < s.config.born) continue;
         const int lost = lost_track(s, k);
-        s.track[k].number = lost >= 0 ? s.track[lost].number : ++s.born;
-        if (lost < 0) continue;
-        s.track[k].hits += s.track[lost].hits;
-        remove(s, lost);
+        if (lost >= 0)
+            take_over(s, k, lost);
+        else
+            s.track[k].number = ++s.born;
     }
 }
 
-/// A mode that moved stood beside itself while the models held samples from before and behind: the younger of two has a number
-/// of its own when the older one is not seen any more, and takes its number.
+/// A mode that jumps stands at both places while the models hold samples from before and after. When it is not seen at the old
+/// one any more, the track at the new one takes its number.
 void marry(okid_tracks& s) {
     for (int j = s.count - 1; j >= 0; --j) {
         const okid_track_t old = s.track[j];
@@ -255,16 +262,12 @@ void marry(okid_tracks& s) {
         double least = alone;
         for (int k = 0; k < s.count; ++k) {
             const okid_track_t& one = s.track[k];
-            if (one.number <= old.number || one.misses > 0) continue;
-            if (one.hits - old.misses > std::min(old.hits, s.config.dies))
-                continue; // stood beside it for long: another mode
+            const bool another = one.hits - old.misses > std::min(old.hits, s.config.dies); // stood beside it for long
+            if (one.number <= old.number || one.misses > 0 || another) continue;
             const double d = distance_of_track(s, k, j);
             if (d < least) least = d, best = k;
         }
-        if (best < 0) continue;
-        s.track[best].number = old.number;
-        s.track[best].hits += old.hits;
-        remove(s, j);
+        if (best >= 0) take_over(s, best, j);
     }
 }
 

@@ -85,7 +85,7 @@ void a_hum_is_no_mode() {
         std::vector<listed_mode> listed = {driven.mode, {50, 0.0005, 1, 1, {1}, true}};
         hammer_test test({driven}, listed[1], size);
         test.work.context.verdicts = {{true, 0.8, {}}, {true, 0.8, {}}};
-        doubt_scattered(listed, test.options.hits, sample_rate, test.work);
+        doubt_scattered(test.options.hits, sample_rate, test.work.set, listed, test.work.context.verdicts);
         TEST_ASSERT_TRUE(listed[0].in_model && test.work.context.verdicts[0].confident);
         TEST_ASSERT_TRUE(test.work.context.verdicts[0].why.empty());
         TEST_ASSERT_FALSE(listed[1].in_model || test.work.context.verdicts[1].confident);
@@ -105,7 +105,7 @@ void one_hit_a_place_says_nothing_against_a_mode() {
         single.set.add("", test.work.set.rows(test.work.set.records[r]), count);
         hits.push_back(test.options.hits[r]);
     }
-    doubt_scattered(listed, hits, sample_rate, single);
+    doubt_scattered(hits, sample_rate, single.set, listed, single.context.verdicts);
     TEST_ASSERT_TRUE(listed[0].in_model && listed[1].in_model);
 }
 
@@ -117,7 +117,7 @@ void hits_of_other_places_say_nothing_against_modes() {
     hammer_test test({first, second}, {50, 0.0005, 1, 1, {1}, false}, 0);
     for (int& place : test.options.hits) place = 1;
     test.work.context.verdicts = {{true, 0.8, {}}, {true, 0.8, {}}};
-    doubt_scattered(listed, test.options.hits, sample_rate, test.work);
+    doubt_scattered(test.options.hits, sample_rate, test.work.set, listed, test.work.context.verdicts);
     TEST_ASSERT_TRUE(listed[0].in_model && listed[1].in_model);
 }
 

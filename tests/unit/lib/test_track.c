@@ -195,7 +195,6 @@ static void a_jump_is_followed_by_the_shape(void) {
     TEST_ASSERT_EQUAL_INT(3, number[2]);
 }
 
-// A change that is known of: no waiting for three hits, and what stood between is nothing.
 /// So many updates of three modes with a fourth at 8 Hz, and so many without the one at 10 Hz. @return number of the one at 8 Hz
 static int stood_beside(int both, int alone, int kind) {
     settle();
@@ -230,6 +229,7 @@ static void a_mode_that_stood_beside_itself_keeps_its_number(void) {
     TEST_ASSERT_EQUAL_INT(4, stood_beside(120, 60, 0)); // a mode of its own, for as long as tracks live
 }
 
+// A change that is known of: no waiting for three hits, and what stood between is nothing.
 static void an_announced_jump(void) {
     settle();
     for (int k = 0; k < 2; ++k) { // of samples from before and after

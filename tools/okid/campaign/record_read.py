@@ -143,20 +143,25 @@ def _of_file(spec: CampaignSpec, kind: str, path: Path) -> tuple[NDArray[Any], f
     return record.columns(list(spec.channels.names), str(path)), temperature
 
 
+def _missing(samples: Real) -> NDArray[np.bool_] | None:
+    """The rows in which a number is missing, None = none."""
+    absent = ~np.all(np.isfinite(samples), axis=1)
+    return absent if np.any(absent) else None
+
+
 def _as_codes(spec: CampaignSpec, name: str, samples: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.bool_] | None]:
     """The samples as the accumulator takes them; which are missing, None = none. Auto takes them as they are, and does
     without a channel that has no number."""
     codes = spec.channels.codes
     if spec.identification.method == "auto":
-        known = np.isfinite(samples)
-        alive = known.any(axis=0)
+        if samples.dtype.kind != "f":
+            return samples, None
+        alive = np.isfinite(samples).any(axis=0)
         if not np.any(alive):
             raise InputError(f"{name}: holds no number in any row")
-        absent = ~np.all(known[:, alive], axis=1)
-        return samples, absent if np.any(absent) else None
+        return samples, _missing(samples[:, alive])
     if samples.dtype.kind == "f":
-        absent = ~np.all(np.isfinite(samples), axis=1)
-        missing = absent if np.any(absent) else None
+        missing = _missing(samples)
         if not codes:
             return np.ascontiguousarray(samples, dtype=np.float64), missing
         whole = _rounded(spec, name, samples, missing)
